@@ -7,7 +7,7 @@
 use super::super::causes::{Cause, Certainty};
 use super::super::questions::{Content, Question};
 use super::super::simulation::{Rules, simulate};
-use super::super::{Asked, Asking, Diagnosis, TOLERANCES};
+use super::super::{ALLOWED, Asked, Asking, Diagnosis, TOLERANCES};
 use super::ends;
 use crate::exchange::peers::PeerRequest;
 use crate::exchange::peers::wire::errors;
@@ -53,8 +53,10 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     for (row, question) in flights.iter().step_by((flights.len() / FLIGHTS).max(1)).take(FLIGHTS) {
         let mut error = |parts| in_parts(asking, &question.problem, row.rtol?, parts);
         let [Some(whole), Some(few), Some(many)] = PARTS.map(&mut error) else { continue };
-        asked += 1;
-        if many > LEFT * whole {
+        // Where the outcome alone is wrong there is nothing to fall.
+        let is_wrong = whole > ALLOWED * row.rtol?;
+        asked += usize::from(is_wrong);
+        if !is_wrong || many > LEFT * whole {
             continue;
         }
         let steep = if many <= POWER * few { Some(PARTS[1]) } else { (few <= POWER * whole).then_some(PARTS[0]) };
