@@ -1,5 +1,6 @@
-//! Is there a step that is never undercut, or a tolerance? One flight in shorter and shorter times, and at tighter and tighter
-//! tolerances.
+//! Is there a step that is never undercut, or a tolerance, or a tolerance that has a unit? One flight in shorter and shorter times, at
+//! tighter and tighter tolerances, and with other units of length and speed: the relative error of a solver whose tolerance is relative
+//! stays, and that of one with an absolute tolerance of its own falls as the numbers grow.
 
 use super::super::causes::{Cause, Certainty};
 use super::super::{ALLOWED, Asking, Diagnosis, TOLERANCES};
@@ -27,6 +28,14 @@ const FAR: f64 = 100.0;
 const BESIDE: usize = 6;
 const BETWEEN: f64 = 1e-4;
 const SMOOTH: f64 = 0.1;
+
+/// Factors of length and speed, powers of two.
+const SIZES: [f64; 4] = [1.0 / 1024.0, 1.0 / 32.0, 1.0, 32.0];
+/// By how much the error falls at least from one size to the next, and from the first to the last.
+const FALLS: f64 = 3.0;
+const FALLS_IN_ALL: f64 = 1e3;
+/// Part by which a fall of the error with the size differs from the ratio of sizes.
+const SAME_FALL: f64 = 0.05;
 
 /// A flight of a length in a time, nearly, with two terms.
 fn flight(length: f64, duration: f64) -> Problem {
@@ -129,4 +138,37 @@ pub(super) fn smooth_floor(asking: &mut Asking<'_>, found: &Diagnosis) -> Option
         floor.statement
     );
     Some(Cause::plain("tolerance-ignored", statement, Certainty::Likely, floor.explains, floor.of))
+}
+
+/// Whether the error falls as lengths and speeds grow, at one relative tolerance.
+pub(super) fn absolute_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
+    let flights = [(500.0, 0.5), (50.0, 2.0), (2000.0, 0.1)];
+    let mut error_of = |size: f64| {
+        let errors = flights.map(|(static_force, drag)| {
+            let stage = Stage::tunnel(static_force * size, drag / size);
+            let problem = Problem::of_stages(1.0, 100.0 * size, [stage]).with_exit(size);
+            // An exit that is not reached is as wrong as can be.
+            let ends = ends(asking, &problem, &PeerRequest::from_problem(&problem, TOLERANCES[1]));
+            ends.map_or(1.0, |[found, exact]| off(found, exact, problem.impact_speed))
+        });
+        errors.into_iter().fold(f64::EPSILON, f64::max)
+    };
+    let found = SIZES.map(&mut error_of);
+    let [smallest, .., largest] = found[..] else { return None };
+    // The smallest takes the first step that is tried, whatever the tolerance, and the next may too.
+    let falls = found[0] >= found[1] && found[1..].windows(2).all(|pair| pair[0] >= FALLS * pair[1]);
+    // What is added to the equation, and has a unit, falls as the size does: that is no tolerance.
+    let by_size =
+        |(errors, sizes): (&[f64], &[f64])| (errors[0] * sizes[0] / (errors[1] * sizes[1]) - 1.0).abs() < SAME_FALL;
+    if found.windows(2).zip(SIZES.windows(2)).skip(1).all(by_size) {
+        return None;
+    }
+    let statement = format!(
+        "at one relative tolerance the error falls from {smallest:.0e} to {largest:.0e} as the same flight grows {:.0} times \
+         in length and speed: the tolerance, or that of an iteration, is an absolute one, whatever is asked for",
+        SIZES[SIZES.len() - 1] / SIZES[0]
+    );
+    let asked = SIZES.len() * flights.len();
+    (falls && smallest >= FALLS_IN_ALL * largest)
+        .then(|| Cause::plain("absolute-tolerance", statement, Certainty::Likely, asked, asked))
 }
