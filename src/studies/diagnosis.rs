@@ -35,7 +35,7 @@ pub(crate) use self::hypotheses::changed_by_nothing;
 pub use self::hypotheses::{Effect, KnownCause, known_causes};
 #[cfg(feature = "report")]
 pub(crate) use self::ladder::{LADDER, Limit};
-use self::measurements::add_measured;
+use self::measurements::{add_measured, add_weights};
 pub use self::questions::{Content, contents};
 use self::questions::{Question, edge_questions, in_order, questions, slow_questions};
 use self::tolerances::{at_tolerances, row};
@@ -302,6 +302,7 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
     if (found.verdict == Verdict::Failed || is_of_low_order) && !is_named {
         add_measured(&mut asking, all, &mut found);
     }
+    add_weights(&mut asking, &mut found);
     found
 }
 

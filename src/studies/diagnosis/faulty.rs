@@ -1,5 +1,6 @@
 //! Solvers that are wrong on purpose: does a diagnosis say of each what is wrong with it?
 
+mod linearised;
 mod series;
 mod several;
 mod stepping;

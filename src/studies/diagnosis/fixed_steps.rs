@@ -607,6 +607,13 @@ struct Lowering {
 const LOWERS: &[Lowering] = &[
     Lowering {
         id: "drag-lagged",
+        contents: &[Content::Drag],
+        place: "where there is drag, and not with viscosity alone",
+        of_one: ": its V², or a derivative of it, is that of another time",
+        of_more: ": its V² is not that of the scheme's stage",
+    },
+    Lowering {
+        id: "drag-lagged",
         contents: &[Content::Drag, Content::Viscosity],
         place: "where the force depends on V",
         of_one: "",

@@ -6,7 +6,7 @@
 //! - Of steps: the first of a scheme that takes a tolerance (`first_step`), exits over many steps (`within_step`), failing flights in
 //!   ever shorter parts (`long_steps`), and a step or a tolerance that is never undercut or has a unit (`bounds`).
 //! - Of ends: whether they lie on the path (`events`).
-//! - Of fixed steps: one that lands on its exit (`one_step`), and one after another (`several_steps`).
+//! - Of fixed steps: one that lands on its exit (`one_step`, `step_errors`), and one after another (`several_steps`, `multistep`).
 //! - Each stage by itself, from the state that the solver lists at its start (`stage_by_stage`).
 
 mod bounds;
@@ -15,10 +15,12 @@ mod drag;
 mod events;
 mod first_step;
 mod long_steps;
+mod multistep;
 mod one_step;
 mod scaling;
 mod several_steps;
 mod stage_by_stage;
+mod step_errors;
 mod within_step;
 
 use self::stage_by_stage::ByStages;
@@ -82,6 +84,7 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
         let is_refuted = |known: &str| match cause.id.as_str() {
             "clock" | "weights" => known.starts_with("event-time-"),
             "tolerance-ignored" => known == "single-precision",
+            "scheme-coefficient" => known == "drag-lagged",
             _ => false,
         };
         found.causes.retain(|known| !["unknown", "first-order-scheme"].contains(&&*known.id) && !is_refuted(&known.id));
@@ -121,6 +124,17 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
     }
 }
 
+/// Puts a wrong weight of a scheme of several steps in place of a factor of the time: where the weights of x and V add up to another number
+/// than one, the path is right, in another time.
+pub(super) fn add_weights(asking: &mut Asking<'_>, found: &mut Diagnosis) {
+    if found.peer.fixed_step
+        && found.causes.first().is_some_and(|cause| cause.id == "unit:time")
+        && let Some(cause) = several_steps::changed(asking)
+    {
+        found.causes = vec![cause];
+    }
+}
+
 /// What questions made for it show of the solver of `found`.
 pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
     let anew = kept(asking, all, found);
@@ -128,15 +142,18 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         return anew;
     }
     if found.peer.fixed_step {
-        // Where the limit is wrong, so is the force, and the step tells nothing of the scheme.
+        // Where the limit is wrong, so is the force, and the step tells nothing of the scheme but what no force explains.
         if FEW * found.counts.failed > found.counts.asked {
-            return None;
+            return several_steps::changed(asking);
         }
         let claimed = found.orders.iter().filter_map(|order| order.formal_order).reduce(f64::max);
         let claimed = claimed.unwrap_or(LEAST_ORDER);
         return several_steps::measured(asking, claimed)
             .or_else(|| one_step::measured(asking, claimed))
-            .or_else(|| within_step::measured(asking, true));
+            .or_else(|| step_errors::measured(asking, claimed))
+            .or_else(|| several_steps::later(asking, claimed))
+            .or_else(|| within_step::measured(asking, true))
+            .or_else(|| step_errors::later(asking, claimed));
     }
     clock::measured(asking, all, found)
         .or_else(|| clock::weights(asking))

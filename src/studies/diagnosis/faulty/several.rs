@@ -9,11 +9,17 @@ const HALVINGS: usize = 100;
 const STEPS_MAX: usize = 1_000_000;
 const ITERATIONS_MAX: usize = 100;
 
+/// The weights of Adams and Bashforth's scheme of order 3, the newest first, and of Moulton's, that of the new slope first.
+pub(super) const ADAMS: [f64; 3] = [23.0 / 12.0, -16.0 / 12.0, 5.0 / 12.0];
+pub(super) const MOULTON: [f64; 3] = [5.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0];
+
 /// How a step of so many seconds is made, from the states at its start and at the starts of those before it, the newest first.
 #[derive(Clone, Copy)]
 pub(super) enum Scheme {
     /// Adams and Bashforth's, with these weights, the newest first, and whether the first two steps are Euler's.
     Adams([f64; 3], bool),
+    /// Adams and Moulton's corrector behind Bashforth's of order 3, with these weights, that of the new slope first.
+    Corrected([f64; 3]),
     /// The implicit midpoint rule, iterated until V changes by less than this part of it.
     Midpoint(f64),
 }
@@ -52,6 +58,16 @@ impl Scheme {
         let now = states[states.len() - 1];
         match self {
             Self::Midpoint(tolerance) => midpoint(law, mass, now, h, tolerance),
+            Self::Corrected([new, rest @ ..]) if states.len() >= 3 => {
+                let ahead_by = |weights: &[f64], slopes: &[[f64; 2]]| {
+                    let sum = |i| weights.iter().zip(slopes).map(|(weight, slope)| weight * slope[i]).sum();
+                    ahead(now, h, std::array::from_fn(sum))
+                };
+                let slopes: Vec<_> = states.iter().rev().take(3).map(|at| slope(law, mass, *at)).collect();
+                let foreseen = ahead_by(&ADAMS, &slopes);
+                ahead_by(&[new, rest[0], rest[1]], &[slope(law, mass, foreseen), slopes[0], slopes[1]])
+            }
+            Self::Corrected(_) => classical(law, mass, now, h),
             Self::Adams(_, true) if states.len() < 3 => ahead(now, h, slope(law, mass, now)),
             Self::Adams(..) if states.len() < 3 => classical(law, mass, now, h),
             Self::Adams(weights, _) => {

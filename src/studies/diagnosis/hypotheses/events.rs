@@ -89,6 +89,82 @@ fn crater_of_one_force(problem: &Problem, found: &mut Simulated, by_energy: bool
     }
 }
 
+/// The stage behind the crater, of static force and drag alone, by its formulas.
+struct Tunnel {
+    start: f64,
+    /// V² at its start, by the spring of the crater: below zero where the flight rests there.
+    square: f64,
+    /// p/M and 2 q/M.
+    deceleration: f64,
+    rate: f64,
+}
+
+impl Tunnel {
+    fn behind_crater(problem: &Problem) -> Option<Self> {
+        let [crater, law, ..] = &problem.stages[..] else { return None };
+        let square = problem.impact_speed.powi(2) - crater.stiffness * crater.end.powi(2) / problem.mass;
+        let [deceleration, rate] = [law.static_force, 2.0 * law.drag].map(|term| term / problem.mass);
+        let is_plain = law.stiffness == 0.0 && law.viscosity == 0.0 && deceleration > 0.0 && rate >= 0.0;
+        (problem.crater == Some(0) && is_plain).then_some(Self { start: crater.end, square, deceleration, rate })
+    }
+
+    /// The depth at rest.
+    fn rest(&self) -> f64 {
+        let way = match self.rate {
+            0.0 => 0.5 * self.square / self.deceleration,
+            rate => (0.5 * rate * self.square / self.deceleration).ln_1p() / rate,
+        };
+        self.start + way
+    }
+
+    /// V at a depth.
+    fn velocity(&self, depth: f64) -> f64 {
+        let way = depth - self.start;
+        let lost = match self.rate {
+            0.0 => -2.0 * self.deceleration * way,
+            rate => 2.0 * self.deceleration / rate * (-rate * way).exp_m1(),
+        };
+        (self.square * (-self.rate * way).exp() + lost).sqrt()
+    }
+
+    /// The time that it takes to slow down from a velocity to rest.
+    fn time_to_rest(&self, velocity: f64) -> f64 {
+        let root = (0.5 * self.rate / self.deceleration).sqrt();
+        if root == 0.0 { velocity / self.deceleration } else { (root * velocity).atan() / (root * self.deceleration) }
+    }
+}
+
+/// The flight where no rest is looked for in the crater: its depth, or V at an exit before it, is that by the formula for the tunnel, and its
+/// time there counts from V = 0.
+fn rest_by_tunnel(problem: &Problem, found: &mut Simulated) {
+    let Some(tunnel) = Tunnel::behind_crater(problem).filter(|_| found.stage == 0 && found.end.velocity <= 0.0) else {
+        return;
+    };
+    found.end.depth = tunnel.rest();
+    if found.end.depth > problem.exit_depth {
+        let velocity = tunnel.velocity(problem.exit_depth);
+        let time = found.end.time - tunnel.time_to_rest(velocity);
+        found.end = State { time, depth: problem.exit_depth, velocity };
+    }
+}
+
+/// The flight where no exit is looked for in the crater: time and velocity are those of the tunnel, taken back to it.
+fn exit_by_tunnel(problem: &Problem, found: &mut Simulated) {
+    let Some(tunnel) = Tunnel::behind_crater(problem) else { return };
+    if found.stage > 0 || problem.exit_depth >= tunnel.start || found.end.depth < problem.exit_depth {
+        return;
+    }
+    let frequency = (problem.stages[0].stiffness / problem.mass).sqrt();
+    found.end = if tunnel.square <= 0.0 {
+        State { time: FRAC_PI_2 / frequency, depth: problem.impact_speed / frequency, velocity: 0.0 }
+    } else {
+        let (speed, velocity) = (tunnel.square.sqrt(), tunnel.velocity(problem.exit_depth));
+        let early = tunnel.time_to_rest(velocity) - tunnel.time_to_rest(speed);
+        let time = (frequency * tunnel.start).atan2(speed) / frequency - early;
+        State { time, depth: problem.exit_depth, velocity }
+    };
+}
+
 /// The velocity at `depth` in a stage, as if it had no term but those of `KEPT`: p, s, r and q are its bits from the first on.
 fn of_terms<const KEPT: u8>(&Passage { problem, index, start }: &Passage<'_>, depth: f64) -> f64 {
     let way = depth - start.depth;
@@ -134,6 +210,22 @@ fn extrapolated(at: &Passage<'_>, end: State, from: Option<State>, is_even: bool
     }
     let there = square.sqrt();
     State { time: time + 2.0 * way / (velocity + there), depth: end.depth, velocity: there }
+}
+
+fn exit_from_each_start(problem: &mut Problem) {
+    let seen = |index: usize| {
+        Some(problem.start_of(index) + problem.exit_depth).filter(|exit| *exit <= problem.stages[index].end)
+    };
+    problem.exit_depth = (0..problem.stages.len()).find_map(seen).unwrap_or(f64::INFINITY);
+}
+
+/// Stages that the exit cuts are left out, and the next one acts from their start on.
+fn leave_out_cut_stages(problem: &mut Problem) {
+    let exit = problem.exit_depth;
+    if problem.stages[0].end > exit {
+        problem.crater = None;
+    }
+    problem.stages.retain(|law| law.end <= exit || law.end.is_infinite());
 }
 
 fn exit_at_start_of_last(problem: &mut Problem) {
@@ -317,11 +409,18 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "exit-misplaced",
         "the exit is counted from the start of each stage",
         Parameter::None,
-        &[Change::Problem(|p, _| {
-            let seen =
-                |index: usize| Some(p.start_of(index) + p.exit_depth).filter(|exit| *exit <= p.stages[index].end);
-            p.exit_depth = (0..p.stages.len()).find_map(seen).unwrap_or(f64::INFINITY);
-        })],
+        &[Change::Problem(|p, _| exit_from_each_start(p))],
+    ),
+    of(
+        "exit-misplaced",
+        "the exit is counted from the start of each stage, and its depth is reported right",
+        Parameter::None,
+        &[
+            Change::Problem(|p, _| exit_from_each_start(p)),
+            Change::Report(|p, found, _| {
+                right_exit(found, found.end.depth >= p.exit_depth, p.exit_depth - p.start_of(found.stage));
+            }),
+        ],
     ),
     of(
         "exit-misplaced",
@@ -366,6 +465,12 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Problem(|p, _| p.exit_depth = f64::INFINITY)],
     ),
     of(
+        "stage-left-out",
+        "a stage whose end lies beyond the exit is left out, and the next one acts in its place",
+        Parameter::None,
+        &[Change::Problem(|p, _| leave_out_cut_stages(p))],
+    ),
+    of(
         "exit-last-stage-only",
         "the exit is looked for in the last stage alone, and seen as soon as that is entered",
         Parameter::None,
@@ -380,6 +485,18 @@ pub(super) static FAULTS: &[Hypothesis] = &[
                 p.exit_depth = f64::INFINITY;
             }
         })],
+    ),
+    of(
+        "exit-first-stage-missed",
+        "no exit is looked for in the crater: time and V at one are those of the tunnel taken back to it",
+        Parameter::None,
+        &[Change::Report(|p, found, _| exit_by_tunnel(p, found))],
+    ),
+    of(
+        "rest-missed",
+        "no rest is looked for in the crater: the depth of one is that by the formula for the tunnel, with V² below zero behind the crater",
+        Parameter::None,
+        &[Change::Report(|p, found, _| rest_by_tunnel(p, found))],
     ),
     of(
         "exit-first-stage-missed",

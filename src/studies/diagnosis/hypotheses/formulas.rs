@@ -53,10 +53,10 @@ fn from_the_start<const KIND: u8>(problem: &mut Problem) {
     }
 }
 
-/// Rate of decay g (1/s) and square of the frequency w² (1/s²) of every stage of stiffness and viscosity as `of` has them.
+/// Rate of decay g (1/s) and square of the frequency w² (1/s²) of every stage of stiffness, with viscosity or without, as `of` has them.
 fn with_rates(problem: &mut Problem, of: impl Fn(f64, f64) -> (f64, f64)) {
     let mass = problem.mass;
-    for law in problem.stages.iter_mut().filter(|law| is_of_kind(law, DAMPED)) {
+    for law in problem.stages.iter_mut().filter(|law| is_of_kind(law, DAMPED) || is_of_kind(law, SPRING)) {
         let decay = 0.5 * law.viscosity / mass;
         let (decay, square) = of(decay, law.stiffness / mass - decay * decay);
         let stiffness = mass * (decay * decay + square);
@@ -119,6 +119,12 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Problem(|p, n| {
             with_rates(p, |decay, square| (decay, square + (1.0 - n * n) * decay * decay));
         })],
+    ),
+    of(
+        "damping-border",
+        "stages of stiffness, with viscosity or without, are all taken for underdamped: w² is the size of s/M - (r/2M)²",
+        Parameter::None,
+        &[Change::Problem(|p, _| with_rates(p, |decay, square| (decay, square.abs())))],
     ),
     of(
         "damping-border",

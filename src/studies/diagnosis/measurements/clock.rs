@@ -71,6 +71,15 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         flights.iter().map(|[found, exact]| (found.velocity - exact.velocity).abs()).fold(0.0, f64::max) / ROW_SPEED;
     let far = rises.iter().filter(|rise| rise.abs() > OF_PATH * of_path).count() as f64;
     if far >= SHOWN_BY * rises.len() as f64 && smooth >= SHOWN_BY * rises.len() as f64 {
+        // At one speed every rule is right.
+        let coasting = Problem::of_stages(1.0, ROW_SPEED, [Stage::free()]).with_exit(1.0);
+        let at_one_speed = ends(asking, &coasting, &PeerRequest::from_problem(&coasting, TOLERANCES[0]))?;
+        if is_wrong(&at_one_speed) {
+            return said(
+                "the time alone is wrong, also where there is no force, and changes smoothly from exit to exit: the clock goes on by other \
+                 lengths than those of the steps",
+            );
+        }
         return said(
             "the time alone is wrong, and changes smoothly from exit to exit: it is summed over the steps by a rule of a lower order than \
              that of the path",

@@ -176,7 +176,7 @@ fn kick_of_step_asked(asking: &mut Asking<'_>) -> Option<f64> {
 }
 
 /// The end of a flight within one step, which is the same whatever the step asked for.
-fn landed(asking: &mut Asking<'_>, problem: &Problem, _: f64) -> Option<State> {
+pub(super) fn landed(asking: &mut Asking<'_>, problem: &Problem, _: f64) -> Option<State> {
     let is_same = |a: f64, b: f64| (a - b).abs() <= LANDED * a.abs();
     let ends = STEPS.map(|step| {
         let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(problem, TOLERANCES[0]) };

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::causes::{Cause, Certainty};
 use super::super::{Asking, TOLERANCES, end_of};
+use super::multistep::{BASHFORTH, Steps, changed_number};
 use crate::exchange::peers::PeerRequest;
 use crate::physics::{Problem, Stage, State};
 
@@ -18,9 +19,11 @@ const SIZES: [f64; 2] = [0.1, 0.05];
 /// Steps that are looked at, and the first that a start does not reach.
 const STEPS: usize = 10;
 const STARTED: usize = 4;
-/// Parts of a step by which two exits lie behind its end: both must give one state there. Else they are tried this much nearer to it.
+/// Parts of a step by which two exits lie behind its end: both must give one state there. Else they are tried nearer to it, by these
+/// factors: where the steps themselves are inconsistent, so is what is interpolated between them.
 pub(super) const BEHIND: [f64; 2] = [0.1, 0.15];
-const NEARER: f64 = 0.1;
+const NEARER: [f64; 2] = [1.0, 0.1];
+const NEARER_OF_INCONSISTENT: [f64; 2] = [1.0, 0.001];
 /// By how much two values of V at the end of a step may differ, over the square of its size. An interpolation by a chord exceeds both;
 /// a last step of order 1, which an iteration that ends at once makes of every step, exceeds the first alone.
 const ONE_STATE: f64 = 1e-3;
@@ -31,17 +34,17 @@ const ON_TIME: f64 = 1e-11;
 /// Difference of two factors of V that are the same, and of two weights.
 const ONE_FACTOR: f64 = 1e-7;
 const ONE_WEIGHT: f64 = 2e-3;
-/// Slopes from which a step is made at most, and the highest order of [`adams`].
+/// Slopes from which a step is made at most.
 const KEPT_MAX: usize = 4;
 /// By how much the power of an error may differ from an integer.
 const NEAR: f64 = 0.2;
 
-/// Sizes of steps (powers of ten) from which an iteration shows where it ends, and the half that `(V1/V0 - 1 + z)/z²` nears.
-const POWERS: [i32; 2] = [-5, -1];
-const HALF: f64 = 0.5;
-/// By how much it may differ where steps are right, and must where they are not.
-const RIGHT: f64 = 0.1;
-const WRONG: f64 = 0.25;
+/// Powers of the size of a step, and sizes (powers of ten) that show where its iteration ends: under `V' = -r V` the term of this power
+/// is there in steps of every size, or in the longer ones alone.
+const TERMS: [(i32, [i32; 2]); 2] = [(2, [-5, -1]), (3, [-4, -1])];
+/// Part of a term by which it may differ where steps are right, and must where they are not.
+const RIGHT: f64 = 0.2;
+const WRONG: f64 = 0.5;
 /// Halvings of a bracket of sizes.
 const HALVINGS: usize = 8;
 
@@ -63,8 +66,8 @@ pub(super) fn state_at(asking: &mut Asking<'_>, problem: &Problem, [step, time, 
     None
 }
 
-/// The factors by which the first `count` steps of size `size` multiply V.
-fn factors(asking: &mut Asking<'_>, size: f64, count: usize, may_differ: f64) -> Option<Vec<f64>> {
+/// The first `count` steps of size `size`.
+fn steps(asking: &mut Asking<'_>, (size, count): (f64, usize), may_differ: f64, nearer: [f64; 2]) -> Option<Steps> {
     // M = 1 kg, r = 1 kg/s, V0 = 1 m/s: the time is r t/M, and the depth 1 - V.
     let problem = Problem::of_stages(1.0, 1.0, [Stage { viscosity: 1.0, ..Stage::free() }]);
     let mut velocity_behind = |steps: usize, part: f64| {
@@ -73,26 +76,20 @@ fn factors(asking: &mut Asking<'_>, size: f64, count: usize, may_differ: f64) ->
         Some(found.velocity * (part * size).exp())
     };
     // An interpolant of a step that is wrong is so less near its start.
-    [1.0, NEARER].into_iter().find_map(|nearer| {
-        let mut before = 1.0;
-        let mut factor = |steps: usize| {
+    nearer.into_iter().find_map(|nearer| {
+        let mut velocity = |steps: usize| {
             let [one, other] = BEHIND.map(|part| velocity_behind(steps, nearer * part));
             let (one, other) = (one?, other?);
-            ((one - other).abs() <= may_differ * size * size).then(|| one / std::mem::replace(&mut before, one))
+            ((one - other).abs() <= may_differ * size * size).then_some(one)
         };
-        (1..=count).map(&mut factor).collect()
+        let behind = (1..=count).map(&mut velocity).collect::<Option<Vec<_>>>()?;
+        Some(Steps { size, velocities: std::iter::once(1.0).chain(behind).collect() })
     })
 }
 
 /// The weights of the last slopes, the newest first, if so few of them give all later steps.
-fn weights(factors: &[f64], size: f64) -> Option<Vec<f64>> {
-    let velocities: Vec<f64> = std::iter::once(1.0)
-        .chain(factors.iter().scan(1.0, |velocity, factor| {
-            *velocity *= factor;
-            Some(*velocity)
-        }))
-        .collect();
-    let later = STARTED..factors.len();
+fn weights(Steps { size, velocities }: &Steps) -> Option<Vec<f64>> {
+    let later = STARTED..velocities.len() - 1;
     (1..=KEPT_MAX).find_map(|kept| {
         let slopes = DMatrix::from_fn(later.len(), kept, |row, slope| -size * velocities[STARTED + row - slope]);
         let changes = DVector::from_fn(later.len(), |row, _| velocities[STARTED + row + 1] - velocities[STARTED + row]);
@@ -102,91 +99,133 @@ fn weights(factors: &[f64], size: f64) -> Option<Vec<f64>> {
     })
 }
 
-/// The weights of Adams and Bashforth's scheme of this order, up to four.
-fn adams(order: usize) -> Option<&'static [f64]> {
-    match order {
-        1 => Some(&[1.0]),
-        2 => Some(&[1.5, -0.5]),
-        3 => Some(&[23.0 / 12.0, -16.0 / 12.0, 5.0 / 12.0]),
-        4 => Some(&[55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0]),
-        _ => None,
+/// Slopes of earlier steps with other weights than those of Adams and Bashforth's scheme of the order `claimed`, as a sentence.
+fn other_weights(claimed: f64, [coarse, fine]: &[Steps; 2]) -> Option<String> {
+    let right = BASHFORTH.get((claimed.round() as usize).checked_sub(1)?)?;
+    let (found, fine) = (weights(coarse)?, weights(fine)?);
+    let is_same =
+        |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= ONE_WEIGHT);
+    let falls_short = (0..claimed.round() as i32).any(|power| {
+        let moment: f64 = fine.iter().enumerate().map(|(back, weight)| weight * (-(back as f64)).powi(power)).sum();
+        (moment - 1.0 / f64::from(power + 1)).abs() > 2.0 * KEPT_MAX as f64 * ONE_WEIGHT
+    });
+    let list = |of: &[f64]| of.iter().map(|weight| format!("{weight:.4}")).collect::<Vec<_>>().join(", ");
+    (is_same(&found, &fine) && found.len() > 1 && !is_same(&fine, right) && falls_short).then(|| {
+        format!(
+            "the last slopes have the weights {}, the newest first, where Adams and Bashforth's scheme of order {} has {}",
+            list(&fine),
+            claimed.round(),
+            list(right)
+        )
+    })
+}
+
+/// The steps of both sizes, where later ones multiply V by another number than the first.
+fn unlike_the_first(asking: &mut Asking<'_>, nearer: [f64; 2]) -> Option<[Steps; 2]> {
+    let coarse = steps(asking, (SIZES[0], STEPS), ONE_STATE, nearer)?;
+    let is_as_later = (coarse.factor(0) - coarse.factor(STEPS - 1)).abs() <= ONE_FACTOR;
+    if is_as_later {
+        return None;
     }
+    Some([coarse, steps(asking, (SIZES[1], STEPS), ONE_STATE, nearer)?])
+}
+
+fn of_weights(statement: String) -> Cause {
+    let asked = SIZES.len() * STEPS;
+    Cause::plain("scheme-coefficient", statement, Certainty::Certain, asked, asked)
+}
+
+/// One number of a known scheme that is another, which no force explains.
+pub(super) fn changed(asking: &mut Asking<'_>) -> Option<Cause> {
+    changed_number(&unlike_the_first(asking, NEARER_OF_INCONSISTENT)?, STARTED).map(of_weights)
+}
+
+/// The order of a step, by its errors at both sizes.
+fn order_of(both: &[Steps; 2], step: usize) -> Option<f64> {
+    let [one, other] = both.each_ref().map(|of| of.factor(step) * of.size.exp() - 1.0);
+    let power = (one / other).abs().log2();
+    ((power - power.round()).abs() <= NEAR).then(|| power.round() - 1.0)
 }
 
 /// What steps show of a scheme that should have the order `claimed`.
 pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
-    if let Some(cause) = iteration(asking) {
+    if let Some(cause) = iteration(asking, claimed) {
         return Some(cause);
     }
-    let [Some(coarse), Some(fine)] = SIZES.map(|size| factors(asking, size, STEPS, ONE_STATE)) else { return None };
+    let both = unlike_the_first(asking, NEARER)?;
+    let order = |step| order_of(&both, step);
+    let falls_short = order(STEPS - 1).is_none_or(|later| later < claimed);
+    let changed = || if falls_short { changed_number(&both, STARTED) } else { None };
+    if let Some(statement) = other_weights(claimed, &both).or_else(changed) {
+        return Some(of_weights(statement));
+    }
     let asked = SIZES.len() * STEPS;
-    // The order of a step, by its errors at both sizes.
-    let order = |step: usize| {
-        let [one, other] = [(&coarse, SIZES[0]), (&fine, SIZES[1])].map(|(of, size)| of[step] * size.exp() - 1.0);
-        let power = (one / other).abs().log2();
-        ((power - power.round()).abs() <= NEAR).then(|| power.round() - 1.0)
-    };
-    let is_as_later = |step: usize| (coarse[step] - coarse[STEPS - 1]).abs() <= ONE_FACTOR;
-    if is_as_later(0) {
-        return None;
-    }
-    let [coarse_weights, fine_weights] = [weights(&coarse, SIZES[0]), weights(&fine, SIZES[1])];
-    if let (Some(found), Some(fine)) = (coarse_weights, fine_weights)
-        && let Some(right) = adams(claimed.round() as usize)
-        && found.len() == fine.len()
-        && found.len() > 1
-        && found.iter().zip(&fine).all(|(one, other)| (one - other).abs() <= ONE_WEIGHT)
-    {
-        let is_right = right.len() == found.len()
-            && found.iter().zip(right).all(|(found, right)| (found - right).abs() <= ONE_WEIGHT);
-        let falls_short = (0..claimed.round() as i32).any(|power| {
-            let moment: f64 = fine.iter().enumerate().map(|(back, weight)| weight * (-(back as f64)).powi(power)).sum();
-            (moment - 1.0 / f64::from(power + 1)).abs() > 2.0 * KEPT_MAX as f64 * ONE_WEIGHT
-        });
-        if !is_right && falls_short {
-            let list = |of: &[f64]| of.iter().map(|weight| format!("{weight:.4}")).collect::<Vec<_>>().join(", ");
-            let statement = format!(
-                "the last slopes have the weights {}, the newest first, where Adams and Bashforth's scheme of order {} has {}",
-                list(&fine),
-                claimed.round(),
-                list(right)
-            );
-            return Some(Cause::plain("scheme-coefficient", statement, Certainty::Certain, asked, asked));
-        }
-    }
     let (first, later) = (order(0)?, order(STEPS - 1)?);
     let started = (0..STEPS).take_while(|step| order(*step) == Some(first)).count();
     // A start of one order less does no harm, since few steps have it; one of none is a kick.
-    (first >= 1.0 && first + 2.0 <= later.min(claimed) && started < STEPS).then(|| {
+    if first >= 1.0 && first + 2.0 <= later.min(claimed) && started < STEPS {
         let statement = format!(
             "the first {started} steps of a flight have order {first}, and later ones {later}: a scheme of several steps is started by one \
              of too low an order"
         );
-        Cause::plain("start-low-order", statement, Certainty::Certain, asked, asked)
-    })
+        return Some(Cause::plain("start-low-order", statement, Certainty::Certain, asked, asked));
+    }
+    None
+}
+
+/// The lower order of the later steps, and their first wrong term.
+pub(super) fn later(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
+    let both = unlike_the_first(asking, NEARER)?;
+    let later = order_of(&both, STEPS - 1).filter(|order| (1.0..claimed).contains(order))?;
+    let power = later as i32 + 1;
+    let [coarse, fine] = both.each_ref().map(|of| (of.factor(STEPS - 1) - (-of.size).exp()) / (-of.size).powi(power));
+    let right = (1..=power).fold(1.0, |product, k| product / f64::from(k));
+    // Of smaller steps, less what the error has in the next power.
+    let found = right + 2.0 * fine - coarse;
+    let statement = format!(
+        "later steps under V' = z V/h give V the term {found:.3} z^{power}, where order {power} has {right:.3} z^{power}: a weight of the \
+         scheme is wrong"
+    );
+    let asked = SIZES.len() * STEPS;
+    let cause = Cause::plain("scheme-coefficient", statement, Certainty::Likely, asked, asked);
+    Some(Cause { factor: Some(found / right), ..cause })
+}
+
+/// By what part of it one step's term of this `power` is off.
+fn term_off(asking: &mut Asking<'_>, power: i32, size: f64) -> Option<f64> {
+    let found = steps(asking, (size, 1), ONE_STATE_OF_ITERATION, NEARER)?.factor(0);
+    let (mut term, mut before) = (1.0, 0.0);
+    for k in 1..=power {
+        before += term;
+        term *= -size / f64::from(k);
+    }
+    Some(((found - before) / term - 1.0).abs())
 }
 
 /// Whether steps that change V little have another order than those that change it more: an iteration within them ends too early.
-fn iteration(asking: &mut Asking<'_>) -> Option<Cause> {
-    let mut second = |size: f64| {
-        let change = factors(asking, size, 1, ONE_STATE_OF_ITERATION)?[0] - 1.0 + size;
-        Some((change / (size * size) - HALF).abs())
-    };
-    let sizes: Vec<f64> = (POWERS[0]..=POWERS[1]).map(|power| 10f64.powi(power)).collect();
-    let off: Vec<f64> = sizes.iter().map(|size| second(*size)).collect::<Option<_>>()?;
-    let wrong = off.iter().take_while(|off| **off >= WRONG).count();
-    if wrong < 2 || wrong == off.len() || off[wrong..].iter().any(|off| *off > RIGHT) {
-        return None;
+fn iteration(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
+    for (power, [least, greatest]) in TERMS.into_iter().filter(|(power, _)| f64::from(*power) <= claimed) {
+        let sizes: Vec<f64> = (least..=greatest).map(|power| 10f64.powi(power)).collect();
+        let off: Vec<f64> = sizes.iter().map(|size| term_off(asking, power, *size)).collect::<Option<_>>()?;
+        if off.iter().all(|off| *off <= RIGHT) {
+            continue;
+        }
+        let wrong = off.iter().take_while(|off| **off >= WRONG).count();
+        if wrong < 2 || wrong == off.len() || off[wrong..].iter().any(|off| *off > RIGHT) {
+            return None;
+        }
+        let (mut low, mut high) = (sizes[wrong - 1], sizes[wrong]);
+        for _ in 0..HALVINGS {
+            let middle = (low * high).sqrt();
+            if term_off(asking, power, middle)? >= WRONG { low = middle } else { high = middle }
+        }
+        let statement = format!(
+            "a step that changes V by a part of {low:.1e} or less has order {}, and one that changes it by more has a higher order: an \
+             iteration within the step ends once it changes little",
+            power - 1
+        );
+        let asked = off.len() + HALVINGS;
+        return Some(Cause::plain("iteration-loose", statement, Certainty::Certain, asked, asked));
     }
-    let (mut low, mut high) = (sizes[wrong - 1], sizes[wrong]);
-    for _ in 0..HALVINGS {
-        let middle = (low * high).sqrt();
-        if second(middle)? >= WRONG { low = middle } else { high = middle }
-    }
-    let statement = format!(
-        "a step that changes V by a part of {low:.1e} or less has order 1, and one that changes it by more has a higher order: an iteration \
-         within the step ends once it changes little"
-    );
-    let asked = off.len() + HALVINGS;
-    Some(Cause::plain("iteration-loose", statement, Certainty::Certain, asked, asked))
+    None
 }

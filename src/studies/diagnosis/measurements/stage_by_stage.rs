@@ -15,7 +15,7 @@ use super::super::{Asking, Diagnosis, QUANTITIES, TOLERANCES, end_of, request};
 use crate::exchange::peers::wire::{conditioning, errors};
 use crate::exchange::peers::{PeerAnswer, PeerRequest};
 use crate::integrators::{Detail, Integrator, Taylor};
-use crate::physics::{Concrete, CraterStiffness, Criterion, EventKind, Outcome, Problem, Scene, Stage, State};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Event, EventKind, Outcome, Problem, Scene, Stage, State};
 use crate::studies::verdict::Verdict;
 
 /// Relative errors over the condition up to which a passage is right, and from which it is wrong: of a solver that takes a tolerance,
@@ -34,6 +34,8 @@ const MOST: f64 = 0.8;
 const SOME: f64 = 0.25;
 /// Right passages elsewhere, over the wrong ones, that are far more.
 const FAR_MORE: usize = 5;
+/// The same for a size of stages to be what is wrong, and not their steps.
+const FAR_MORE_THAN_OF_STEPS: usize = 10;
 /// What a condition costs, without a number and with one, in parts of all right passages that it holds for.
 const PRICE: f64 = 0.01;
 const PRICE_OF_NUMBER: f64 = 0.04;
@@ -124,7 +126,7 @@ pub(super) const OF_TERM: [(&str, &str); 4] = [
 /// A number of a passage: what it is, its unit, and itself.
 type Number = (&'static str, &'static str, fn(&Passage<'_>) -> f64);
 
-static NUMBERS: [Number; 27] = [
+static NUMBERS: [Number; 28] = [
     ("the smaller force at its ends", " N", |at| at.forces()[0].min(at.forces()[1])),
     ("the greater force at its ends", " N", |at| at.forces()[0].max(at.forces()[1])),
     ("V at its start", " m/s", |at| at.from.velocity),
@@ -146,6 +148,7 @@ static NUMBERS: [Number; 27] = [
         at.law.stiffness.abs() * at.distance().powi(2) / (at.mass * at.from.velocity.powi(2))
     }),
     ("r²/(4 s M)", "", |at| at.law.viscosity.powi(2) / (4.0 * at.law.stiffness.abs() * at.mass)),
+    ("4 s M - r²", " kg²/s²", |at| 4.0 * at.law.stiffness * at.mass - at.law.viscosity.powi(2)),
     ("its share of the time so far", "", |at| at.end.time / (at.from.time + at.end.time)),
     ("the diameter", " m", |at| at.of_concrete(|concrete| concrete.diameter)),
     ("the strength", " Pa", |at| at.of_concrete(|concrete| concrete.strength)),
@@ -320,8 +323,8 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
             failing.push(question);
         }
         let asked = PeerRequest { dt_s: row.dt_s, ..request(question, TOLERANCES[TOLERANCES.len() - 1]) };
-        let Ok(answer) = asking.ask(&asked) else { continue };
-        passages.extend(passages_of(question, asking.reads_scene, &answer, bounds));
+        let Ok((answer, through)) = with_ends(asking, question, &asked) else { continue };
+        passages.extend(passages_of(question, asking.reads_scene, (&answer, through), bounds));
         let (late, right): (Vec<_>, Vec<_>) = unlisted_passages_of(question, asking.reads_scene, &answer, bounds)
             .into_iter()
             .partition(|passage| passage.is_supposed);
@@ -338,8 +341,9 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         if asking.is_gone || count(&passages) >= ENOUGH {
             break;
         }
-        let Ok(answer) = asking.ask(&request(question, TOLERANCES[TOLERANCES.len() - 1])) else { continue };
-        passages.extend(passages_of(question, asking.reads_scene, &answer, bounds));
+        let asked = request(question, TOLERANCES[TOLERANCES.len() - 1]);
+        let Ok((answer, through)) = with_ends(asking, question, &asked) else { continue };
+        passages.extend(passages_of(question, asking.reads_scene, (&answer, through), bounds));
     }
     let (wrong, right): (Vec<&Passage<'_>>, Vec<&Passage<'_>>) =
         passages.iter().partition(|passage| passage.is_wrong());
@@ -371,7 +375,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let times = factor.map_or_else(String::new, |factor| format!(", {factor:.6} times the right one,"));
     let said: Vec<String> = conditions.iter().map(ToString::to_string).collect();
     let statement = format!(
-        "the flight through a stage, from the state listed at its start, has a wrong {what}{times} {} {}: {} of {inside} such \
+        "the flight through a stage, from the solver's state at its start, has a wrong {what}{times} {} {}: {} of {inside} such \
          passages, and none of the {elsewhere} others",
         if is_what { "where" } else { "in part of those where" },
         said.join(" and "),
@@ -398,7 +402,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let is_of_kinds = !has_number && !conditions.iter().all(Condition::is_of_an_end);
     // Passages of one question follow each other.
     let shown_by = wrong.chunk_by(|one, next| std::ptr::eq(one.question, next.question)).count();
-    let is_told_apart = elsewhere >= FAR_MORE * wrong.len();
+    let is_told_apart = elsewhere >= FAR_MORE_THAN_OF_STEPS * wrong.len();
     Some(ByStages { cause: Cause { factor, ..cause }, is_of_kinds, is_told_apart, shown_by })
 }
 
@@ -439,7 +443,7 @@ fn of_term(
     let (id, what) = OF_TERM[term];
     let changed = if factor == 0.0 { format!("without {what}") } else { format!("with {factor:.6} times {what}") };
     let statement = format!(
-        "the flight through a stage, from the state listed at its start, is that {changed}{place}: {count} of {} wrong passages",
+        "the flight through a stage, from the solver's state at its start, is that {changed}{place}: {count} of {} wrong passages",
         wrong.len()
     );
     let explained = explained_of(failing, wrong);
@@ -458,11 +462,28 @@ fn one_factor(ratios: impl Iterator<Item = f64>) -> Option<f64> {
     (same as f64 >= MOST * ratios.len() as f64).then_some(middle)
 }
 
-/// The passages of an `answer` to `problem` of which it is plain whether they are right.
+/// The answer to `asked`, and how the flight goes through its stages: where it lists no events, their ends are asked for as exits.
+fn with_ends(asking: &mut Asking<'_>, question: &Question, asked: &PeerRequest) -> Result<(PeerAnswer, Way), String> {
+    let mut answer = asking.ask(asked)?;
+    if asking.reads_scene || !answer.events.is_empty() {
+        return Ok((answer, Way::Through));
+    }
+    let problem = &question.problem;
+    let end_of_flight = answer.depth_m.min(problem.exit_depth);
+    for (index, law) in problem.stages.iter().enumerate().take_while(|(_, law)| law.end < end_of_flight) {
+        let up_to = problem.clone().with_exit(law.end);
+        let request = PeerRequest { dt_s: asked.dt_s, ..PeerRequest::from_problem(&up_to, asked.rtol) };
+        let state = end_of(&asking.ask(&request)?).state;
+        answer.events.push(Event { kind: EventKind::StageEnd(index), state });
+    }
+    Ok((answer, Way::Exit))
+}
+
+/// The passages of an `answer` to `problem` of which it is plain whether they are right; `through` is how it goes through a stage.
 fn passages_of<'a>(
     question: &'a Question,
     reads_scene: bool,
-    answer: &PeerAnswer,
+    (answer, through): (&PeerAnswer, Way),
     bounds: [f64; 2],
 ) -> Vec<Passage<'a>> {
     let mut passages = Vec::new();
@@ -481,7 +502,8 @@ fn passages_of<'a>(
         }
         let found = listed.unwrap_or(last);
         let judged = judged(question, index, [from, found], boundary, bounds);
-        passages.extend(judged.map(|passage| Passage { scene, ..passage }));
+        let way = |passage: &Passage<'_>| if passage.way == Way::Through { through } else { passage.way };
+        passages.extend(judged.map(|passage| Passage { scene, way: way(&passage), ..passage }));
         if listed.is_none() {
             break;
         }
