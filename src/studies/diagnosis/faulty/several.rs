@@ -22,6 +22,8 @@ pub(super) enum Scheme {
     Corrected([f64; 3]),
     /// The implicit midpoint rule, iterated until V changes by less than this part of it.
     Midpoint(f64),
+    /// Gauss's of two slopes, iterated until `h` times what they change is less than this part of V.
+    Gauss(f64),
 }
 
 fn slope(law: &Stage, mass: f64, at: State) -> [f64; 2] {
@@ -53,11 +55,30 @@ fn midpoint(law: &Stage, mass: f64, now: State, h: f64, tolerance: f64) -> State
     State { time: now.time + h, depth: now.depth + h * middle, velocity: 2.0 * middle - now.velocity }
 }
 
+fn gauss(law: &Stage, mass: f64, now: State, h: f64, tolerance: f64) -> State {
+    let root = 3f64.sqrt() / 6.0;
+    let weights = [[0.25, 0.25 - root], [0.25 + root, 0.25]];
+    let mut slopes = [slope(law, mass, now); 2];
+    let sum = |[b1, b2]: [f64; 2], slopes: &[[f64; 2]; 2]| {
+        ahead(now, h, std::array::from_fn(|i| b1 * slopes[0][i] + b2 * slopes[1][i]))
+    };
+    for _ in 0..ITERATIONS_MAX {
+        let next = weights.map(|weights| slope(law, mass, sum(weights, &slopes)));
+        let before = std::mem::replace(&mut slopes, next);
+        let change = (0..2).map(|stage| (slopes[stage][1] - before[stage][1]).abs()).fold(0.0, f64::max);
+        if h * change <= tolerance * now.velocity {
+            break;
+        }
+    }
+    sum([0.5, 0.5], &slopes)
+}
+
 impl Scheme {
     fn step(self, law: &Stage, mass: f64, states: &[State], h: f64) -> State {
         let now = states[states.len() - 1];
         match self {
             Self::Midpoint(tolerance) => midpoint(law, mass, now, h, tolerance),
+            Self::Gauss(tolerance) => gauss(law, mass, now, h, tolerance),
             Self::Corrected([new, rest @ ..]) if states.len() >= 3 => {
                 let ahead_by = |weights: &[f64], slopes: &[[f64; 2]]| {
                     let sum = |i| weights.iter().zip(slopes).map(|(weight, slope)| weight * slope[i]).sum();

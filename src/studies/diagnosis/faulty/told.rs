@@ -703,6 +703,18 @@ const TOLD: &[Told] = &[
         says: "passed | ",
     },
     Told {
+        what: "nothing, by the same, measured",
+        solver: || Linear::Times(1.0).solver(),
+        asked: Claiming(2.0),
+        says: "",
+    },
+    Told {
+        what: "a Jacobian lacks the drag, and no order is claimed",
+        solver: || Linear::WithoutDrag.solver(),
+        asked: Questions(120),
+        says: "passed | drag-lagged, likely: the order falls to 1 where there is drag, and not with viscosity alone: its V², or a derivative of it, is that of another time",
+    },
+    Told {
         what: "the linear part of a force has the factor 1.0002",
         solver: || Linear::Times(1.0002).solver(),
         asked: Claiming(2.0),
@@ -731,6 +743,18 @@ const TOLD: &[Told] = &[
         solver: || Scheme::Midpoint(1e-3).solver(),
         asked: Claiming(2.0),
         says: "iteration-loose, certain: a step that changes V by a part of 2.0e-3 or less has order 1, and one that changes it by more has a higher order: an iteration within the step ends once it changes little",
+    },
+    Told {
+        what: "an iteration ends once V changes by a millionth, behind the second pass at least",
+        solver: || Scheme::Gauss(1e-6).solver(),
+        asked: Claiming(4.0),
+        says: "iteration-loose, certain: a step that changes V by a part of 1.1e-3 or less has order 2, and one that changes it by more has a higher order: an iteration within the step ends once it changes little",
+    },
+    Told {
+        what: "an iteration of two slopes goes on until they stay",
+        solver: || Scheme::Gauss(1e-15).solver(),
+        asked: Claiming(4.0),
+        says: "",
     },
     Told {
         what: "an iteration goes on until V stays",

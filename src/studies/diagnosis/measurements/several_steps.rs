@@ -154,9 +154,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     }
     let both = unlike_the_first(asking, NEARER)?;
     let order = |step| order_of(&both, step);
-    let falls_short = order(STEPS - 1).is_none_or(|later| later < claimed);
-    let changed = || if falls_short { changed_number(&both, STARTED) } else { None };
-    if let Some(statement) = other_weights(claimed, &both).or_else(changed) {
+    if let Some(statement) = other_weights(claimed, &both).or_else(|| changed_number(&both, STARTED)) {
         return Some(of_weights(statement));
     }
     let asked = SIZES.len() * STEPS;
