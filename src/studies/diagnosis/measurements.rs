@@ -98,27 +98,30 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
     }
     if let Some(ByStages { cause, is_of_kinds, is_told_apart, shown_by }) = by_stages {
         found.causes.retain(|known| known.id != "unknown" || cause.certainty == Certainty::Possible);
-        let is_of_every_kind = |known: &Cause| OF_EVERY_KIND.iter().chain(&SYMPTOMS).any(|id| *id == known.id);
+        let is_likely = cause.certainty == Certainty::Likely;
+        let acts_everywhere = |known: &Cause| OF_EVERY_KIND.contains(&known.id.as_str());
+        let is_of_every_kind = |known: &Cause| acts_everywhere(known) || SYMPTOMS.contains(&known.id.as_str());
         // Steps that are too long are so everywhere.
         let is_of_size = found.causes.first().is_some_and(|known| known.id == "steps-too-long") && is_told_apart;
-        let says_more = is_of_kinds || (found.peer.fixed_step || is_of_size) && cause.certainty == Certainty::Likely;
+        let is_of_some = is_of_kinds || found.peer.fixed_step || is_of_size;
+        let says_more_than =
+            |known: &Cause| is_likely && is_of_some && is_of_every_kind(known) || is_of_kinds && acts_everywhere(known);
         // What acts in stages of every kind does not where only some kinds are wrong.
         if is_of_kinds {
-            for known in found.causes.iter_mut().filter(|known| OF_EVERY_KIND.contains(&known.id.as_str())) {
+            for known in found.causes.iter_mut().filter(|known| acts_everywhere(known)) {
                 known.certainty = known.certainty.max(Certainty::Possible);
             }
         }
         // One that explains half as many questions, or fewer, says less, and so does one that fits a single answer.
         let explains_few = |known: &Cause| {
             known.certainty == cause.certainty
-                && cause.certainty == Certainty::Likely
+                && is_likely
                 && known.id != "steps-too-long"
                 && (is_of_kinds || !is_of_every_kind(known) || measured.as_ref() != Some(&known.id))
                 && (2 * known.explains <= cause.explains || known.explains == 1 && shown_by > 1)
         };
-        let goes_behind = |known: &Cause| {
-            known.certainty > cause.certainty || says_more && is_of_every_kind(known) || explains_few(known)
-        };
+        let goes_behind =
+            |known: &Cause| known.certainty > cause.certainty || says_more_than(known) || explains_few(known);
         let place = usize::from(found.causes.first().is_some_and(|known| !goes_behind(known)));
         found.causes.insert(place, cause);
     }

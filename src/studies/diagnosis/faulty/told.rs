@@ -734,9 +734,9 @@ const TOLD: &[Told] = &[
     },
     Told {
         what: "static force and spring are applied before viscosity and drag",
-        solver: || Linear::OneByOne.solver(),
-        asked: Claiming(2.0),
-        says: "scheme-coefficient, likely: one step of a time h has an error of 4.987e-1 h^2 in V, and so the order 1 in place of 2, under a static force and viscosity, V' = -1 - V: each is applied by itself, one after the other",
+        solver: || Linear::OneByOne.solver().claiming(2.0),
+        asked: Questions(120),
+        says: "failed | scheme-coefficient, likely: one step of a time h has an error of 4.987e-1 h^2 in V, and so the order 1 in place of 2, under a static force and viscosity, V' = -1 - V: each is applied by itself, one after the other",
     },
     Told {
         what: "an iteration ends once V changes by a thousandth",

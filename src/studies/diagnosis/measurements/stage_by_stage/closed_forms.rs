@@ -18,6 +18,8 @@ const MOST: f64 = 0.5;
 const MOST_OF_SUPPOSED: f64 = 0.9;
 /// Relative difference of what a formula gives from what is answered.
 const FITS: f64 = 1e-7;
+/// Passages that a slip explains over the right ones that contradict it, at least.
+const FAR_MORE_THAN_RIGHT: usize = 10;
 /// The same of a right passage: less is no contradiction.
 const CONTRADICTS: f64 = 1e-5;
 
@@ -361,22 +363,23 @@ impl Kind {
         })
     }
 
-    /// The passages of `wrong` that `slip` explains, if those are enough, and none of `right` that ends alike contradicts.
+    /// How the passages of `wrong` end that `slip` explains, and how many it says nothing of, if those are enough, and hardly one of `right`
+    /// that ends alike contradicts.
     fn explained_by(
         &self,
         read: &Read,
         slip: &Slip,
         wrong: &[&Passage<'_>],
         right: &[&Passage<'_>],
-    ) -> Option<Vec<Way>> {
+    ) -> Option<(Vec<Way>, usize)> {
         let part = if wrong.iter().any(|passage| passage.is_supposed) { MOST_OF_SUPPOSED } else { MOST };
         let may_leave = wrong.len() - (part * wrong.len() as f64).ceil() as usize;
-        let (mut ways, mut left) = (Vec::new(), 0);
+        let (mut ways, mut left, mut silent) = (Vec::new(), 0, 0);
         for passage in wrong {
             match self.explains(read, slip, passage) {
                 Some(true) => ways.push(passage.way),
                 Some(false) => left += 1,
-                None => {}
+                None => silent += 1,
             }
             if left > may_leave {
                 return None;
@@ -384,7 +387,9 @@ impl Kind {
         }
         let contradicts =
             |passage: &&&Passage<'_>| ways.contains(&passage.way) && self.is_contradicted(read, slip, passage);
-        (ways.len() >= ENOUGH && !right.iter().any(|passage| contradicts(&passage))).then_some(ways)
+        // For short ways a solver may have a series.
+        let is_right = ways.len() >= FAR_MORE_THAN_RIGHT * right.iter().filter(contradicts).count();
+        (ways.len() >= ENOUGH && is_right).then_some((ways, silent))
     }
 
     /// What `slip` changes, of passages that end by `ways`.
@@ -417,7 +422,7 @@ pub(super) struct Explained {
     pub statement: String,
     /// Wrong passages that it explains.
     pub count: usize,
-    /// All of them; of those that are supposed to be wrong, those of its kind.
+    /// All of which it says something; of those that are supposed to be wrong, those of its kind.
     pub of: usize,
 }
 
@@ -437,11 +442,11 @@ pub(super) fn explained(wrong: &[&Passage<'_>], right: &[&Passage<'_>]) -> Optio
             continue;
         }
         for slip in (0..read.formulas.len()).flat_map(|place| kind.slips(read, place)) {
-            if let Some(ways) = kind.explained_by(read, &slip, &of_wrong, &of_right)
+            if let Some((ways, silent)) = kind.explained_by(read, &slip, &of_wrong, &of_right)
                 && best.as_ref().is_none_or(|best| ways.len() > best.count)
             {
                 let is_supposed = of_wrong.iter().all(|passage| passage.is_supposed);
-                let of = if is_supposed { of_wrong.len() } else { wrong.len() };
+                let of = if is_supposed { of_wrong.len() } else { wrong.len() - silent };
                 best = Some(Explained { statement: kind.said(read, &slip, &ways), count: ways.len(), of });
             }
         }

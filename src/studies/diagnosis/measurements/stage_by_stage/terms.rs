@@ -28,9 +28,10 @@ pub(super) struct Factored {
 /// The term with the factor that gives most of `wrong`.
 pub(super) fn factored(wrong: &[&Passage<'_>]) -> Option<Factored> {
     let of_term = |term: usize| {
-        let mut factors: Vec<f64> = wrong.iter().filter_map(|passage| fitted(passage, term)).collect();
+        let is_one = |from: f64, to: f64| (to - from).abs() <= FITS * to.abs().max(1.0);
+        let factors = wrong.iter().filter_map(|passage| fitted(passage, term));
+        let mut factors: Vec<f64> = factors.filter(|factor| !is_one(1.0, *factor)).collect();
         factors.sort_by(f64::total_cmp);
-        let is_one = |from: f64, to: f64| to - from <= FITS * to.abs().max(1.0);
         let runs = (0..factors.len()).map(|first| {
             let count = factors[first..].iter().take_while(|factor| is_one(factors[first], **factor)).count();
             Factored { term, factor: factors[first + count / 2], count }
