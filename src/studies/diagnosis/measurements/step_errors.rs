@@ -29,8 +29,8 @@ const ONE_STATE: f64 = 1e-3;
 /// How near to the end of a step its state is asked for, over [`BEHIND`].
 const NEARER: f64 = 0.1;
 
-/// The flight of 1 kg from 1 m/s: p, s, r and q of its force (SI), its velocity (m/s) after a time (s), its depth (m), and what is wrong where its errors
-/// alone have a lower power.
+/// The flight of 1 kg from 1 m/s: p, s, r and q of its force (SI), its velocity (m/s) and its depth (m) after a time (s), and what is
+/// wrong where its errors alone have a lower power.
 struct Motion {
     terms: [f64; 4],
     velocity: fn(f64) -> f64,
@@ -86,12 +86,15 @@ fn power(asking: &mut Asking<'_>, motion: &Motion) -> Option<(f64, f64)> {
     ((found - whole).abs() <= NEAR).then(|| (whole, of_short / short.powf(whole)))
 }
 
-/// The power of the error of the step under drag alone that starts at [`LATER`].
-fn power_later(asking: &mut Asking<'_>) -> Option<f64> {
+/// The power of the error of the step under drag alone that starts at a time (s).
+fn power_under_drag(asking: &mut Asking<'_>, start: f64) -> Option<f64> {
     let law = Stage { drag: 1.0, ..Stage::free() };
     let problem = Problem::of_stages(1.0, 1.0, [law]);
     // V at a time, from exits a little behind it, by the right flight.
     let mut velocity = |time: f64, size: f64| {
+        if time == 0.0 {
+            return Some(problem.impact_speed);
+        }
         let [one, other] = BEHIND.map(|part| {
             let late = NEARER * part * size;
             let found = state_at(asking, &problem, [size, time + late, (time + late).ln_1p()])?;
@@ -101,7 +104,7 @@ fn power_later(asking: &mut Asking<'_>) -> Option<f64> {
         ((one - other).abs() <= ONE_STATE * size * size).then_some(one)
     };
     let [coarse, fine] = LATER_SIZES.map(|size| {
-        let (before, behind) = (velocity(LATER, size)?, velocity(LATER + size, size)?);
+        let (before, behind) = (velocity(start, size)?, velocity(start + size, size)?);
         Some(behind - 1.0 / (1.0 / before + size))
     });
     let power = (coarse? / fine?).abs().log2();
@@ -110,11 +113,9 @@ fn power_later(asking: &mut Asking<'_>) -> Option<f64> {
 
 /// The first motion under which a step has a lower order than `claimed`, where the ones before it do not.
 pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
-    let mut right = Vec::new();
-    for motion in &MOTIONS {
+    for (right, motion) in MOTIONS.iter().enumerate() {
         let (power, factor) = power(asking, motion)?;
         if power > claimed {
-            right.push(motion);
             continue;
         }
         let few_digits =
@@ -124,7 +125,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
             power - 1.0,
             motion.said
         );
-        let asked = SIZES.len() * (right.len() + 1);
+        let asked = SIZES.len() * (right + 1);
         return Some(Cause::plain("scheme-coefficient", statement, Certainty::Likely, asked, asked));
     }
     None
@@ -132,12 +133,13 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
 
 /// Whether steps under drag alone have a lower order later than at impact, where they do not under viscosity.
 pub(super) fn later(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
-    let later = power_later(asking).filter(|power| *power <= claimed)?;
+    let [first, later] = [0.0, LATER].map(|start| power_under_drag(asking, start));
+    let later = later.filter(|power| *power <= claimed && first.is_some_and(|first| first > claimed))?;
     let statement = format!(
         "under drag alone the first step has the order {claimed}, and later ones {}: what a step takes from the drag, such as a linear part, \
          is that of the start of the stage",
         later - 1.0
     );
-    let asked = 2 * BEHIND.len() * LATER_SIZES.len();
+    let asked = 3 * BEHIND.len() * LATER_SIZES.len();
     Some(Cause::plain("drag-lagged", statement, Certainty::Likely, asked, asked))
 }
