@@ -122,7 +122,13 @@ fn behind_stage_end(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     };
     let (ended, near, far) = by(landed).or_else(|| by(not_landed))?;
     if let Some((what, [found, right])) = near.first_wrong(claimed) {
-        return if near.is_same_as(&far) && !passes_whole(asking) {
+        let passed = if found.abs() <= SAME { passed_end(asking) } else { None };
+        if passed == Some(Passed::Right) {
+            let statement =
+                "the end of a stage is missed in the step that reaches the exit: that step has the force before it";
+            return certain("stage-end-missed", statement.to_owned());
+        }
+        return if near.is_same_as(&far) && passed != Some(Passed::Whole) {
             let statement =
                 format!("the first step behind the end of a stage has {what} with a factor {found:.6}, not {right}");
             // Where the force is the same on both sides, part of the one before does no harm.
@@ -158,15 +164,25 @@ fn behind_stage_end(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     None
 }
 
-/// Whether a step that passes the end of a stage is taken whole under the force before, here none, and the next one has the new force.
-fn passes_whole(asking: &mut Asking<'_>) -> bool {
+/// How the end of a stage is passed where the exit lies a step behind it.
+#[derive(PartialEq)]
+enum Passed {
+    /// By a step that is taken whole under the force before; the next one has the new force.
+    Whole,
+    /// Rightly.
+    Right,
+}
+
+fn passed_end(asking: &mut Asking<'_>) -> Option<Passed> {
+    const END: f64 = 0.1;
     const STEP: f64 = 0.3;
     const EXIT: f64 = 0.38;
-    let stages = [Stage::free().until(0.1), Stage::tunnel(DECELERATION, 0.0)];
+    let stages = [Stage::free().until(END), Stage::tunnel(DECELERATION, 0.0)];
     let problem = Problem::of_stages(1.0, 1.0, stages).with_exit(EXIT);
     let request = PeerRequest { dt_s: Some(STEP), ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
-    let behind = 1.0 - DECELERATION * (EXIT - STEP);
-    asking.ask(&request).is_ok_and(|answer| (answer.velocity_m_s - behind).abs() <= 0.1 * (1.0 - behind))
+    let lost = (1.0 - asking.ask(&request).ok()?.velocity_m_s) / DECELERATION;
+    let is_over = |way: f64| (lost - way).abs() <= 0.1 * way;
+    if is_over(EXIT - STEP) { Some(Passed::Whole) } else { is_over(EXIT - END).then_some(Passed::Right) }
 }
 
 /// By how much V falls with the step asked for, over the deceleration, where time and depth do not depend on it.
