@@ -151,10 +151,16 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         }
         let claimed = found.orders.iter().filter_map(|order| order.formal_order).reduce(f64::max);
         let claimed = claimed.unwrap_or(LEAST_ORDER);
-        return several_steps::measured(asking, claimed)
+        if let Some(cause) = several_steps::iteration(asking, claimed) {
+            return Some(cause);
+        }
+        let steps = several_steps::unlike_the_first(asking, several_steps::NEARER);
+        return steps
+            .as_ref()
+            .and_then(|steps| several_steps::measured(steps, claimed))
             .or_else(|| one_step::measured(asking, claimed))
             .or_else(|| step_errors::measured(asking, claimed))
-            .or_else(|| several_steps::later(asking, claimed))
+            .or_else(|| several_steps::later(steps.as_ref()?, claimed))
             .or_else(|| within_step::measured(asking, true))
             .or_else(|| step_errors::later(asking, claimed));
     }

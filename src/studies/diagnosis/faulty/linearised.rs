@@ -70,3 +70,49 @@ impl Linear {
         Some(now)
     }
 }
+
+/// How the end of a stage is passed by the scheme with the right linear part.
+#[derive(Clone, Copy)]
+pub(super) enum Passing {
+    /// By a step that is taken whole.
+    Whole,
+    /// By a step that ends there, but for the one that reaches the exit.
+    WholeAtExit,
+}
+
+impl Passing {
+    /// The end of the flight through `problem` by steps of `h` (s), exit and rest by a part of one; `None` where it takes too many.
+    pub(super) fn end(self, problem: &Problem, h: f64) -> Option<State> {
+        let mut now = State::at_impact(problem);
+        for _ in 0..STEPS_MAX {
+            let law = problem.stages.iter().find(|law| now.depth < law.end)?;
+            let ahead = |part: f64| Linear::Times(1.0).ahead(law, problem.mass, now, now.velocity, part);
+            let first = |is_past: &dyn Fn(State) -> bool| {
+                let (mut low, mut high) = (0.0, h);
+                for _ in 0..HALVINGS {
+                    let part = 0.5 * (low + high);
+                    if is_past(ahead(part)) { high = part } else { low = part }
+                }
+                ahead(high)
+            };
+            let next = ahead(h);
+            let is_end = |at: State| at.depth >= problem.exit_depth || at.velocity <= 0.0;
+            if is_end(next) {
+                let end = first(&is_end);
+                let is_exit = end.depth >= problem.exit_depth;
+                return Some(if is_exit {
+                    State { depth: problem.exit_depth, ..end }
+                } else {
+                    State { velocity: 0.0, ..end }
+                });
+            }
+            now = match self {
+                Self::WholeAtExit if next.depth >= law.end => {
+                    State { depth: law.end, ..first(&|at| at.depth >= law.end) }
+                }
+                _ => next,
+            };
+        }
+        None
+    }
+}

@@ -20,6 +20,8 @@ pub(super) enum Scheme {
     Adams([f64; 3], bool),
     /// Adams and Moulton's corrector behind Bashforth's of order 3, with these weights, that of the new slope first.
     Corrected([f64; 3]),
+    /// Backward differences of order 2, with this weight of the new slope.
+    Backward(f64),
     /// The implicit midpoint rule, iterated until V changes by less than this part of it.
     Midpoint(f64),
     /// Gauss's of two slopes, iterated until `h` times what they change is less than this part of V.
@@ -55,6 +57,21 @@ fn midpoint(law: &Stage, mass: f64, now: State, h: f64, tolerance: f64) -> State
     State { time: now.time + h, depth: now.depth + h * middle, velocity: 2.0 * middle - now.velocity }
 }
 
+fn backward(law: &Stage, mass: f64, [now, before]: [State; 2], h: f64, weight: f64) -> State {
+    let of_values = |one: f64, other: f64| (4.0 * one - other) / 3.0;
+    let from =
+        State { depth: of_values(now.depth, before.depth), velocity: of_values(now.velocity, before.velocity), ..now };
+    let mut next = now;
+    for _ in 0..ITERATIONS_MAX {
+        let [dx, dv] = slope(law, mass, next).map(|slope| weight * slope);
+        let last = std::mem::replace(&mut next, State { time: now.time + h, ..ahead(from, h, [dx, dv]) });
+        if next.velocity == last.velocity && next.depth == last.depth {
+            break;
+        }
+    }
+    next
+}
+
 fn gauss(law: &Stage, mass: f64, now: State, h: f64, tolerance: f64) -> State {
     let root = 3f64.sqrt() / 6.0;
     let weights = [[0.25, 0.25 - root], [0.25 + root, 0.25]];
@@ -88,7 +105,10 @@ impl Scheme {
                 let foreseen = ahead_by(&ADAMS, &slopes);
                 ahead_by(&[new, rest[0], rest[1]], &[slope(law, mass, foreseen), slopes[0], slopes[1]])
             }
-            Self::Corrected(_) => classical(law, mass, now, h),
+            Self::Backward(weight) if states.len() >= 2 => {
+                backward(law, mass, [now, states[states.len() - 2]], h, weight)
+            }
+            Self::Corrected(_) | Self::Backward(_) => classical(law, mass, now, h),
             Self::Adams(_, true) if states.len() < 3 => ahead(now, h, slope(law, mass, now)),
             Self::Adams(..) if states.len() < 3 => classical(law, mass, now, h),
             Self::Adams(weights, _) => {

@@ -14,7 +14,7 @@ use super::super::{
     Asking, Cause, Counts, Diagnosis, Plan, QuantityOrder, Question, Solver, Subject, Verdict, by_questions,
     questions_to,
 };
-use super::linearised::Linear;
+use super::linearised::{Linear, Passing};
 use super::series::{RIGHT_SERIES, Series};
 use super::several::{ADAMS, MOULTON, Scheme};
 use super::stepping::{CLASSICAL, Placed, RIGHT, Stepping};
@@ -688,7 +688,7 @@ const TOLD: &[Told] = &[
         what: "a corrector of order 3 adds the slope that it must take off",
         solver: || Scheme::Corrected([MOULTON[0], MOULTON[1], -MOULTON[2]]).solver().claiming(3.0),
         asked: Questions(120),
-        says: "failed | scheme-coefficient, certain: the weight of slope 2, the newest being 1, is 0.0833, not -0.0833, in the corrector of order 3 behind a predictor of order 3",
+        says: "failed | scheme-coefficient, certain: the weight of slope 2 (the newest is 1) is 0.0833, not -0.0833, in the corrector of order 3 behind a predictor of order 3",
     },
     Told {
         what: "a corrector of order 3 that is right",
@@ -718,7 +718,7 @@ const TOLD: &[Told] = &[
         what: "the linear part of a force has the factor 1.0002",
         solver: || Linear::Times(1.0002).solver(),
         asked: Claiming(2.0),
-        says: "scheme-coefficient, likely: one step of a time h has an error of 9.973e-5 h^2 in V, and so the order 1 in place of 2, under viscosity alone, V' = -V: so small an error is that of a number with too few digits",
+        says: "scheme-coefficient, likely: one step of a time h has an error of 9.973e-5 h^2 in V, and so the order 1 in place of 2, under viscosity alone, V' = -V: so small an error is as that of a number with too few digits",
     },
     Told {
         what: "a Jacobian lacks the drag",
@@ -737,6 +737,44 @@ const TOLD: &[Told] = &[
         solver: || Linear::OneByOne.solver().claiming(2.0),
         asked: Questions(120),
         says: "failed | scheme-coefficient, likely: one step of a time h has an error of 4.987e-1 h^2 in V, and so the order 1 in place of 2, under a static force and viscosity, V' = -1 - V: each is applied by itself, one after the other",
+    },
+    Told {
+        what: "backward differences have half of the new slope, not two thirds",
+        solver: || Scheme::Backward(0.5).solver().claiming(2.0),
+        asked: Questions(120),
+        says: "failed | scheme-coefficient, certain: the weight of the new slope is 0.5000, not 0.6667, in the backward differences of order 2",
+    },
+    Told {
+        what: "backward differences that are right",
+        solver: || Scheme::Backward(2.0 / 3.0).solver(),
+        asked: Claiming(2.0),
+        says: "",
+    },
+    Told {
+        what: "backward differences with a viscosity that grows with the mass",
+        solver: || {
+            stepwise(|problem, h| {
+                let mut problem = problem.clone();
+                let factor = 1.0 + 0.3 * problem.mass / (1.0 + problem.mass);
+                problem.stages.iter_mut().for_each(|law| law.viscosity *= factor);
+                Scheme::Backward(2.0 / 3.0).end(&problem, h)
+            })
+            .claiming(2.0)
+        },
+        asked: Questions(120),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is viscosity-1 (viscosity, exit); `viscosity` stands in 100 % of the failing and 2 % of the passing questions",
+    },
+    Told {
+        what: "a step that passes the end of a stage is taken whole",
+        solver: || stepwise(|problem, h| Passing::Whole.end(problem, h)),
+        asked: Questions(120),
+        says: "passed | stage-end-late, certain: steps do not land on the ends of stages: where the force jumps the order falls to 1",
+    },
+    Told {
+        what: "the end of a stage is missed in the step that reaches the exit",
+        solver: || stepwise(|problem, h| Passing::WholeAtExit.end(problem, h)),
+        asked: Claiming(2.0),
+        says: "stage-end-missed, certain: the end of a stage is missed in the step that reaches the exit: that step has the force before it",
     },
     Told {
         what: "an iteration ends once V changes by a thousandth",

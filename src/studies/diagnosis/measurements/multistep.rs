@@ -68,6 +68,8 @@ pub(super) struct Steps {
     pub size: f64,
     /// The first is that at impact, 1 m/s.
     pub velocities: Vec<f64>,
+    /// By how much `x + V` differs from V0, at most: by nothing, whatever the weights, where both have the same.
+    pub off_path: f64,
 }
 
 impl Steps {
@@ -106,7 +108,7 @@ impl Multistep {
     /// Its numbers in the order of [`Self::left`], and what each is called.
     fn numbers(&self) -> Vec<(f64, String)> {
         let listed = |of: &'static [f64], what: &'static str| {
-            of.iter().enumerate().map(move |(back, number)| (*number, format!("{what} {}", back + 1)))
+            of.iter().enumerate().map(move |(back, number)| (*number, format!("{what} {} (the newest is 1)", back + 1)))
         };
         listed(self.values, "the weight of V")
             .chain(listed(self.slopes, "the weight of slope"))
@@ -124,8 +126,7 @@ impl Multistep {
             let mean = changes.iter().sum::<f64>() / changes.len() as f64;
             let is_one = changes.iter().all(|change| (change - mean).abs() <= ONE_CHANGE * mean.abs());
             let found = right + mean;
-            (is_one && mean.abs() > CHANGED)
-                .then(|| format!("{what}, the newest being 1, is {found:.4}, not {right:.4}, in {}", self.name))
+            (is_one && mean.abs() > CHANGED).then(|| format!("{what} is {found:.4}, not {right:.4}, in {}", self.name))
         })
     }
 }

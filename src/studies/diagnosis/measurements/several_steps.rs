@@ -22,7 +22,7 @@ const STARTED: usize = 4;
 /// Parts of a step by which two exits lie behind its end: both must give one state there. Else they are tried nearer to it, by these
 /// factors: where the steps themselves are inconsistent, so is what is interpolated between them.
 pub(super) const BEHIND: [f64; 2] = [0.1, 0.15];
-const NEARER: [f64; 2] = [1.0, 0.1];
+pub(super) const NEARER: [f64; 2] = [1.0, 0.1];
 const NEARER_OF_INCONSISTENT: [f64; 2] = [1.0, 0.001];
 /// By how much two values of V at the end of a step may differ, over the square of its size. An interpolation by a chord exceeds both;
 /// a last step of order 1, which an iteration that ends at once makes of every step, exceeds the first alone.
@@ -34,6 +34,8 @@ const ON_TIME: f64 = 1e-11;
 /// Difference of two factors of V that are the same, and of two weights.
 const ONE_FACTOR: f64 = 1e-7;
 const ONE_WEIGHT: f64 = 2e-3;
+/// By how much `x + V` may differ from V0 where the force is right.
+const ON_PATH: f64 = 1e-3;
 /// Slopes from which a step is made at most.
 const KEPT_MAX: usize = 4;
 /// By how much the power of an error may differ from an integer.
@@ -70,25 +72,28 @@ pub(super) fn state_at(asking: &mut Asking<'_>, problem: &Problem, [step, time, 
 fn steps(asking: &mut Asking<'_>, (size, count): (f64, usize), may_differ: f64, nearer: [f64; 2]) -> Option<Steps> {
     // M = 1 kg, r = 1 kg/s, V0 = 1 m/s: the time is r t/M, and the depth 1 - V.
     let problem = Problem::of_stages(1.0, 1.0, [Stage { viscosity: 1.0, ..Stage::free() }]);
+    let mut off_path = 0.0_f64;
     let mut velocity_behind = |steps: usize, part: f64| {
         let time = (steps as f64 + part) * size;
         let found = state_at(asking, &problem, [size, time, -(-time).exp_m1()])?;
+        off_path = off_path.max((found.depth + found.velocity - 1.0).abs());
         Some(found.velocity * (part * size).exp())
     };
     // An interpolant of a step that is wrong is so less near its start.
-    nearer.into_iter().find_map(|nearer| {
+    let velocities = nearer.into_iter().find_map(|nearer| {
         let mut velocity = |steps: usize| {
             let [one, other] = BEHIND.map(|part| velocity_behind(steps, nearer * part));
             let (one, other) = (one?, other?);
             ((one - other).abs() <= may_differ * size * size).then_some(one)
         };
         let behind = (1..=count).map(&mut velocity).collect::<Option<Vec<_>>>()?;
-        Some(Steps { size, velocities: std::iter::once(1.0).chain(behind).collect() })
-    })
+        Some(std::iter::once(1.0).chain(behind).collect())
+    })?;
+    Some(Steps { size, velocities, off_path })
 }
 
 /// The weights of the last slopes, the newest first, if so few of them give all later steps.
-fn weights(Steps { size, velocities }: &Steps) -> Option<Vec<f64>> {
+fn weights(Steps { size, velocities, .. }: &Steps) -> Option<Vec<f64>> {
     let later = STARTED..velocities.len() - 1;
     (1..=KEPT_MAX).find_map(|kept| {
         let slopes = DMatrix::from_fn(later.len(), kept, |row, slope| -size * velocities[STARTED + row - slope]);
@@ -121,7 +126,7 @@ fn other_weights(claimed: f64, [coarse, fine]: &[Steps; 2]) -> Option<String> {
 }
 
 /// The steps of both sizes, where later ones multiply V by another number than the first.
-fn unlike_the_first(asking: &mut Asking<'_>, nearer: [f64; 2]) -> Option<[Steps; 2]> {
+pub(super) fn unlike_the_first(asking: &mut Asking<'_>, nearer: [f64; 2]) -> Option<[Steps; 2]> {
     let coarse = steps(asking, (SIZES[0], STEPS), ONE_STATE, nearer)?;
     let is_as_later = (coarse.factor(0) - coarse.factor(STEPS - 1)).abs() <= ONE_FACTOR;
     if is_as_later {
@@ -135,9 +140,11 @@ fn of_weights(statement: String) -> Cause {
     Cause::plain("scheme-coefficient", statement, Certainty::Certain, asked, asked)
 }
 
-/// One number of a known scheme that is another, which no force explains.
+/// One number of a known scheme that is another, which no force explains: whatever the weights, `x + V M/r` stays.
 pub(super) fn changed(asking: &mut Asking<'_>) -> Option<Cause> {
-    changed_number(&unlike_the_first(asking, NEARER_OF_INCONSISTENT)?, STARTED).map(of_weights)
+    let both = unlike_the_first(asking, NEARER_OF_INCONSISTENT)?;
+    let is_of_weights = both.iter().all(|steps| steps.off_path <= ON_PATH);
+    if is_of_weights { changed_number(&both, STARTED).map(of_weights) } else { None }
 }
 
 /// The order of a step, by its errors at both sizes.
@@ -148,13 +155,9 @@ fn order_of(both: &[Steps; 2], step: usize) -> Option<f64> {
 }
 
 /// What steps show of a scheme that should have the order `claimed`.
-pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
-    if let Some(cause) = iteration(asking, claimed) {
-        return Some(cause);
-    }
-    let both = unlike_the_first(asking, NEARER)?;
-    let order = |step| order_of(&both, step);
-    if let Some(statement) = other_weights(claimed, &both).or_else(|| changed_number(&both, STARTED)) {
+pub(super) fn measured(both: &[Steps; 2], claimed: f64) -> Option<Cause> {
+    let order = |step| order_of(both, step);
+    if let Some(statement) = other_weights(claimed, both).or_else(|| changed_number(both, STARTED)) {
         return Some(of_weights(statement));
     }
     let asked = SIZES.len() * STEPS;
@@ -172,9 +175,8 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
 }
 
 /// The lower order of the later steps, and their first wrong term.
-pub(super) fn later(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
-    let both = unlike_the_first(asking, NEARER)?;
-    let later = order_of(&both, STEPS - 1).filter(|order| (1.0..claimed).contains(order))?;
+pub(super) fn later(both: &[Steps; 2], claimed: f64) -> Option<Cause> {
+    let later = order_of(both, STEPS - 1).filter(|order| (1.0..claimed).contains(order))?;
     let power = later as i32 + 1;
     let [coarse, fine] = both.each_ref().map(|of| (of.factor(STEPS - 1) - (-of.size).exp()) / (-of.size).powi(power));
     let right = (1..=power).fold(1.0, |product, k| product / f64::from(k));
@@ -201,7 +203,7 @@ fn term_off(asking: &mut Asking<'_>, power: i32, size: f64) -> Option<f64> {
 }
 
 /// Whether steps that change V little have another order than those that change it more: an iteration within them ends too early.
-fn iteration(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
+pub(super) fn iteration(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     for (power, [least, greatest]) in TERMS.into_iter().filter(|(power, _)| f64::from(*power) <= claimed) {
         let sizes: Vec<f64> = (least..=greatest).map(|power| 10f64.powi(power)).collect();
         let off: Vec<f64> = sizes.iter().map(|size| term_off(asking, power, *size)).collect::<Option<_>>()?;

@@ -1,6 +1,6 @@
 //! Through which stages does a solver go wrong? Each stage is judged by itself, from the state that the solver lists at its start.
 //!
-//! The list of events cuts a flight into passages, one a stage. Where the formula of one kind of stage is wrong, or one below a
+//! The list of events cuts a flight into passages, one a stage; a solver without a list is asked for exits at the ends of stages. Where the formula of one kind of stage is wrong, or one below a
 //! threshold, the wrong passages have something in common: the simplest [`Condition`], or pair of them, that holds for all of them
 //! and for hardly any right one.
 
@@ -473,7 +473,9 @@ fn with_ends(asking: &mut Asking<'_>, question: &Question, asked: &PeerRequest) 
     for (index, law) in problem.stages.iter().enumerate().take_while(|(_, law)| law.end < end_of_flight) {
         let up_to = problem.clone().with_exit(law.end);
         let request = PeerRequest { dt_s: asked.dt_s, ..PeerRequest::from_problem(&up_to, asked.rtol) };
-        let state = end_of(&asking.ask(&request)?).state;
+        // What came so far tells of its stages.
+        let Ok(there) = asking.ask(&request) else { break };
+        let state = end_of(&there).state;
         answer.events.push(Event { kind: EventKind::StageEnd(index), state });
     }
     Ok((answer, Way::Exit))

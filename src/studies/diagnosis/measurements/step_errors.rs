@@ -119,7 +119,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
             continue;
         }
         let few_digits =
-            if factor.abs() < SMALL { ": so small an error is that of a number with too few digits" } else { "" };
+            if factor.abs() < SMALL { ": so small an error is as that of a number with too few digits" } else { "" };
         let statement = format!(
             "one step of a time h has an error of {factor:.3e} h^{power} in V, and so the order {} in place of {claimed}, under {}{few_digits}",
             power - 1.0,

@@ -18,10 +18,10 @@ const MOST: f64 = 0.5;
 const MOST_OF_SUPPOSED: f64 = 0.9;
 /// Relative difference of what a formula gives from what is answered.
 const FITS: f64 = 1e-7;
-/// Passages that a slip explains over the right ones that contradict it, at least.
-const FAR_MORE_THAN_RIGHT: usize = 10;
 /// The same of a right passage: less is no contradiction.
 const CONTRADICTS: f64 = 1e-5;
+/// Passages that a slip explains over the right ones that contradict it, at least.
+const FAR_MORE_THAN_RIGHT: usize = 10;
 
 /// Names in formulas before those that they define.
 const NAMES: [&str; 10] = ["M", "p", "s", "r", "q", "x0", "V0", "L", "T", "V1"];
